@@ -18,7 +18,7 @@ export const ENGLISH = {
   "act-straight": "Set turnout {0} straight", "act-curved": "Set turnout {0} curved", "act-model": "Show its calibration", "act-train": "Show train {0}", "act-line": "Check the link",
   "act-health": "Show the alarms", "end-alarm": "Done", "end-alarm-of": "Done: {0}", "more-alarms": "{0} more alarms",
   "crossing": "level crossing: one train at a time",
-  "crossing-held": "Train {0} and train {1} stand near the level crossing at {2}: neither may start while the other is less than 200 mm from it. Lift one of them, put it further away, then click where it is.",
+  "crossing-held": "Train {0} and train {1} are at rest near the level crossing at {2}: neither may start while the other is less than 200 mm from it. Lift one of them, put it further away, then click where it is.",
   "guide": "The remedy of this alarm", "guide-unknown": "Position of train {0} unknown",
   "guide-look": "Look where the train is; put it back on the track if it has left it.",
   "guide-click": "Click that place on the track below and press `Train {0} is here`. `Other direction` names it for the way the train faces.",
@@ -79,7 +79,7 @@ export const ENGLISH = {
   "truth-mm": "true error (mm)", "did-stop": "stop", "did-move": "move", "did-arrive": "arrive", "did-speed": "speed",
   "did-go": "go", "did-reverse": "reverse", "did-hold": "hold", "did-follow": "follow",
   "now-seeks": "Position unknown: it runs at step {0} until a sensor reports it.", "now-lost": "Position unknown: run it past a sensor, or say where it stands.",
-  "now-rests": "Stands at {0}.", "now-waits": "Stands at {0}; current order: {1}.", "now-runs": "Runs at {0}, step {1}.",
+  "now-rests": "At rest at {0}.", "now-waits": "At rest at {0}; current order: {1}.", "now-runs": "Runs at {0}, step {1}.",
   "now-slows": "Slows down from {0}: stops at {1} ± {2} mm.", "now-does": "Runs at {0}; current order: {1}.", "now-stops": "Runs at {0}; {1}: predicted {2} … {3} mm from the target.", "achieved": "done: {0}",
   "lock": "Lock to this train", "unlock": "Unlock", "lock-hint": "The lock leaves only the throttle, and the train stops when this page is hidden or the phone is put away.",
 

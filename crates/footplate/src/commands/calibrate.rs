@@ -55,8 +55,8 @@ enum Method {
 
 /// Calibrate a train on a layout, or trains from recorded sensor reports.
 ///
-/// With --link, the train is found wherever it stands, driven by a plan that is made as it goes on, and left standing
-/// within the budget: speeds and stops by throttle step, and how sure they are. From recordings: the same motion model of
+/// With --link, Footplate locates the train, drives it by a plan that it makes as it learns, and leaves it at rest
+/// within the budget: speeds and stops by throttle step, with their uncertainties. From recordings: the same motion model of
 /// each train, and beside it the laws that describe its changes of speed, residuals and corrected lengths. Every number has
 /// one standard deviation and the number of measurements behind it.
 #[derive(Args)]

@@ -10,7 +10,7 @@ use clap::{Args, Subcommand};
 
 use super::Outcome;
 
-/// Add what was measured by hand, such as where a train stands by the tape.
+/// Add a measurement by hand, such as the place of rest of a train, measured with a tape.
 #[derive(Args)]
 #[command(after_help = "Example: footplate measure stop --store railway.db --train 24 --at C13+120mm")]
 pub(crate) struct Arguments {

@@ -163,7 +163,7 @@ test("two trains beside one crossing are told why neither may start, and how it 
   // 32 mm short of it, on the other track.
   await say(program, "place 58 at B1+250mm");
   await until(page, () => document.querySelector("#crossings-held").textContent);
-  assert.match(await held(), /^Train 24 and train 58 stand near the level crossing at A1\+94mm: neither may start while .* 200 mm .* click where it is\.$/);
+  assert.match(await held(), /^Train 24 and train 58 are at rest near the level crossing at A1\+94mm: neither may start while .* 200 mm .* click where it is\.$/);
   assert.deepEqual(await findings(page), []);
   await page.screenshot({ path: join(AT, "crossing-held.png") });
   // A command is refused or waits; the remedy of its alarm is the same.

@@ -167,7 +167,7 @@ test("a throttle is locked to its train on a phone, and the train stops when the
     Object.defineProperty(document, "hidden", { value: true, configurable: true });
     document.dispatchEvent(new Event("visibilitychange"));
   });
-  await until(page, () => /^(Slows down from|Stands at)/.test(document.querySelector("#now").textContent));
+  await until(page, () => /^(Slows down from|At rest at)/.test(document.querySelector("#now").textContent));
   await page.evaluate(() => delete document.hidden);
   await page.click("#lock");
   assert.ok(await page.locator("nav").isVisible());

@@ -1,4 +1,4 @@
-//! `footplate measure stop`: where a train stands by the tape, and what that changes.
+//! `footplate measure stop`: adds a place of rest measured with a tape, and shows what that changes.
 
 use std::io::Write;
 use std::path::PathBuf;
