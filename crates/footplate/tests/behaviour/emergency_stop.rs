@@ -136,6 +136,10 @@ impl Served {
 
 impl Drop for Served {
     fn drop(&mut self) {
+        // Without its guardian it would try for ever to stop trains at a board that is gone.
+        if let Some(driving) = child_of(self.child.id()) {
+            signal("KILL", driving);
+        }
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
