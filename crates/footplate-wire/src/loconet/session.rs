@@ -154,14 +154,17 @@ impl Client {
     fn driving(&mut self, now: Timestamp, train: TrainId, step: SpeedStep) -> (Request, Option<Awaited>) {
         let forward = self.dialogue.locomotives.get(train).and_then(|known| known.forward).unwrap_or(true);
         let speed = speed_of(step, self.dialogue.decoder(train)).unwrap_or_default();
-        let awaited = Some(Awaited::Driven(train, speed, forward));
-        let Some(slot) = self.slots.of_mut(train) else { return (Request::Locomotive(train.0), awaited) };
+        let request = self.drive_request(now, train, speed, forward);
+        (request, Some(Awaited::Driven(train, speed, forward)))
+    }
+
+    /// Sets the direction, too, if the slot was last read with another one. A train without a slot gets one first.
+    fn drive_request(&mut self, now: Timestamp, train: TrainId, speed: u8, forward: bool) -> Request {
+        let found = self.slots.of_mut(train).and_then(|slot| Some((slot.number?, slot)));
+        let Some((number, slot)) = found else { return Request::Locomotive(train.0) };
         slot.refreshed = now;
         let direction = (slot.forward != forward).then_some((forward, slot.functions));
-        match slot.number {
-            Some(slot) => (Request::Drive { slot, speed, direction }, awaited),
-            None => (Request::Locomotive(train.0), awaited),
-        }
+        Request::Drive { slot: number, speed, direction }
     }
 
     /// Ends the opening: trains may run.
@@ -217,7 +220,11 @@ impl Protocol for Client {
         self.verify();
     }
 
-    fn send(&mut self, now: Timestamp, next: Outgoing<Awaited>) {
+    fn send(&mut self, now: Timestamp, mut next: Outgoing<Awaited>) {
+        // Slots report more after the first try: the slot itself, or another direction, which only a message of its own sets.
+        if let (2.., Some(Awaited::Driven(train, speed, forward))) = (next.tries, next.awaited) {
+            next.request = self.drive_request(now, train, speed, forward);
+        }
         let request = next.request;
         self.outbox.push(request.messages());
         self.write_waiting(now);

@@ -32,6 +32,25 @@ fn an_unconfirmed_reversal_is_taken_back_at_the_end() {
     assert!(!desk.texts()[stops_at..].contains(&reverses), "{:?}", desk.texts());
 }
 
+/// LocoNet commands the direction by a message of its own, which a stop has only if the slot was read with the other one.
+#[test]
+fn an_obeyed_reversal_without_an_answer_is_taken_back_in_its_slot() {
+    let mut desk = loconet_session::Desk::opened();
+    desk.command(speed(T24, 8));
+    desk.run_for(300);
+    desk.command(speed(T24, 0));
+    desk.run_for(600);
+    desk.command(Command::Reverse { train: T24 });
+    // The station obeys, and its answer is lost with the line.
+    desk.run_for(8);
+    assert!(!desk.station.slots[&1].forward);
+    desk.coming.clear();
+    desk.client.handle_reopened(desk.now);
+    let closing = desk.close(4_000);
+    assert!(closing.is_complete(), "{closing}");
+    assert!(desk.station.slots[&1].forward);
+}
+
 #[test]
 fn a_locomotive_that_the_board_forgot_goes_on_in_the_direction_of_the_session_before() {
     let mut desk = dcc_ex_desk::Desk::opened();

@@ -64,6 +64,10 @@ impl<'l> Teller<'_, 'l> {
             {
                 self.note("neither the program nor its guardian is left".to_owned());
             }
+            (None, Guardian::Dead { .. }) if !is_complete && pair.tried_in_vain() => {
+                let words = "the station never confirmed to a program without a guardian that all is stopped";
+                self.fail(FailureKind::RanOn, words.to_owned());
+            }
             // The program has stopped its trains itself.
             (None, Guardian::Dead { since } | Guardian::Hangs { since, .. }) => {
                 let stopped_at = stopped_at.filter(|_| pair.line.all_stopped());

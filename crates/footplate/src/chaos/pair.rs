@@ -35,6 +35,9 @@ pub(super) enum Guardian {
 
 const FOR_EVER: Timestamp = Timestamp::from_ns(i64::MAX);
 
+/// A person ends a program that still tries to stop its trains so long after its guardian has failed. No line is cut for so long.
+const TRIES_FOR: TimeSpan = TimeSpan::from_ms(120_000);
+
 /// Bytes from one process to the other that it has not read.
 struct Pipe {
     sent: VecDeque<u8>,
@@ -121,6 +124,11 @@ impl<'l> Pair<'l> {
 
     pub(super) const fn guardian(&self) -> Guardian {
         self.guardian
+    }
+
+    /// Whether the program was still trying to stop its trains when a person ended it.
+    pub(super) fn tried_in_vain(&self) -> bool {
+        matches!(self.guardian, Guardian::Dead { since } if self.line.time() - since > TRIES_FOR)
     }
 
     /// Lets everything happen that is due.
@@ -397,7 +405,7 @@ impl Connection for Pair<'_> {
     }
 
     fn gives_up(&self) -> bool {
-        self.life.is_over()
+        self.life.is_over() || self.tried_in_vain()
     }
 
     fn say(&mut self, words: &str) {

@@ -350,8 +350,7 @@ impl<'r, L: Link> Runtime<'r, L> {
     fn release_guardian(&mut self) -> Result<(), Lost> {
         let is_complete = self.session.closing().is_complete();
         if !is_complete && self.link.is_without_guardian() {
-            let lost = "the station has not confirmed that all trains are stopped, which is commanded again"
-                .to_owned();
+            let lost = format!("{}; all of it is commanded again", self.session.closing());
             say!("{lost}");
             return Err(Lost(lost));
         }
