@@ -138,7 +138,7 @@ fn it_stops_there_over_a_network_with_messages_in_parts_and_other_text_between_t
 #[cfg(unix)]
 #[test]
 fn a_board_at_a_pseudo_terminal_is_found() {
-    let board = Standing::with("pty", "20", &["--protocol", "dcc-ex"]);
+    let board = Standing::with("pty", "5", &["--protocol", "dcc-ex"]);
     let doctor = footplate(&["doctor", "--link", &board.address, "--seconds", "20"]);
     assert_eq!(doctor.status, 0, "{}{}", doctor.output, doctor.errors);
     assert!(doctor.output.contains("0 without an answer"), "{}", doctor.output);

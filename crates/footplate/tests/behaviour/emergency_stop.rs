@@ -18,8 +18,12 @@ use crate::guardian::{child_of, signal};
 use crate::station::Standing;
 use crate::uploads::upload;
 
-/// The command that takes the power from the track, which the stop sends.
+/// How the command that stops the train begins, the first that an emergency stop sends.
+const STOP: &[u8] = b"<t 24 0 ";
+/// The command that takes the power from the track, the last that it sends.
 const POWER_OFF: &[u8] = b"<0>";
+/// The end of a command.
+const END: u8 = b'>';
 /// Between two bytes of a slow one.
 const SLOW: Duration = Duration::from_millis(100);
 /// Nothing here takes longer.
@@ -38,19 +42,27 @@ struct Load {
     uploads: usize,
 }
 
-/// Passes bytes between the program and a board, and knows what was said, and when the power was commanded off.
+/// When the commands of emergency stops were on the line.
+#[derive(Clone, Default)]
+struct Stops {
+    trains: Vec<Instant>,
+    power: Vec<Instant>,
+}
+
+/// Passes bytes between the program and a board, and knows what was said, and when trains and power were commanded off.
 pub(crate) struct Tap {
     pub(crate) place: String,
     said: Arc<Mutex<String>>,
-    off: Arc<Mutex<Vec<Instant>>>,
+    stops: Arc<Mutex<Stops>>,
 }
 
 impl Tap {
     pub(crate) fn before(board: &str) -> Self {
         let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
         let place = listener.local_addr().expect("an address").to_string();
-        let (board, off) = (board.to_owned(), Arc::default());
-        let seen: Arc<Mutex<Vec<Instant>>> = Arc::clone(&off);
+        let board = board.to_owned();
+        let stops = Arc::<Mutex<Stops>>::default();
+        let seen = Arc::clone(&stops);
         let said = Arc::<Mutex<String>>::default();
         let text = Arc::clone(&said);
         thread::spawn(move || {
@@ -63,22 +75,29 @@ impl Tap {
                 (station.try_clone().expect("a handle"), program.try_clone().expect("a handle"));
             thread::spawn(move || std::io::copy(&mut answers, &mut back));
             let mut bytes = [0; 4096];
-            let mut last = Vec::new();
+            let mut command = Vec::new();
             while let Ok(count @ 1..) = program.read(&mut bytes) {
-                last.extend_from_slice(&bytes[..count]);
+                let now = Instant::now();
                 text.lock().expect("no panic").push_str(&String::from_utf8_lossy(&bytes[..count]));
-                if last.windows(POWER_OFF.len()).any(|part| part == POWER_OFF) {
-                    seen.lock().expect("no panic").push(Instant::now());
-                    last.clear();
+                for byte in &bytes[..count] {
+                    command.push(*byte);
+                    if *byte == END {
+                        let mut seen = seen.lock().expect("no panic");
+                        match command.trim_ascii_start() {
+                            said if said.starts_with(STOP) => seen.trains.push(now),
+                            POWER_OFF => seen.power.push(now),
+                            _ => {}
+                        }
+                        command.clear();
+                    }
                 }
-                last.drain(..last.len().saturating_sub(POWER_OFF.len() - 1));
                 if station.write_all(&bytes[..count]).is_err() {
                     break;
                 }
             }
             let _ = station.shutdown(Shutdown::Both);
         });
-        Self { place, said, off }
+        Self { place, said, stops }
     }
 
     /// All that the program said.
@@ -86,8 +105,8 @@ impl Tap {
         self.said.lock().expect("no panic").clone()
     }
 
-    fn times(&self) -> Vec<Instant> {
-        self.off.lock().expect("no panic").clone()
+    fn stops(&self) -> Stops {
+        self.stops.lock().expect("no panic").clone()
     }
 }
 
@@ -220,8 +239,13 @@ fn uploading(load: Load, host: &str, ends: &Arc<AtomicBool>) -> [Arc<AtomicUsize
     [computed, refused]
 }
 
-/// How soon each of some emergency stops under a load was on the line.
-fn stops_under(load: Load, name: &str, count: usize) -> Vec<Duration> {
+/// How soon emergency stops under a load were on the line, in order: the command to the train and that to the power.
+struct Took {
+    train: Vec<Duration>,
+    power: Vec<Duration>,
+}
+
+fn stops_under(load: Load, name: &str, count: usize) -> Took {
     let folder = calibrated(name, 7);
     let board = Standing::with("tcp:127.0.0.1:0", "1", &["--protocol", "dcc-ex", "--seed", "7"]);
     let of_board = board.address.strip_prefix("dcc-ex:tcp://").expect(&board.address);
@@ -248,17 +272,24 @@ fn stops_under(load: Load, name: &str, count: usize) -> Vec<Duration> {
         }
     });
     sleep(Duration::from_secs(1));
-    let mut took = Vec::new();
+    let mut took = Took { train: Vec::new(), power: Vec::new() };
     for _ in 0..count {
-        assert!(retried(|| served.post("/api/orders", "{\"line\": \"power on\"}")).contains("202"));
+        // A board is asked for the direction of a train that has not been driven, before that can be stopped.
+        for line in ["power on", "speed 24 1"] {
+            let order = serde_json::json!({ "line": line }).to_string();
+            assert!(retried(|| served.post("/api/orders", &order)).contains("202"));
+        }
         sleep(Duration::from_millis(300));
-        let (before, began) = (tap.times().len(), Instant::now());
+        let (before, began) = (tap.stops().power.len(), Instant::now());
         let answer = served.post("/api/emergency-stop", "{}");
         assert!(answer.contains("202"), "{answer}");
-        while tap.times().len() == before && began.elapsed() < PATIENCE {
+        while tap.stops().power.len() == before && began.elapsed() < PATIENCE {
             sleep(Duration::from_micros(200));
         }
-        took.push(*tap.times().get(before).expect("the power is commanded off") - began);
+        let stops = tap.stops();
+        // A train that is known to be at rest is not commanded again.
+        took.train.extend(stops.trains.iter().find(|at| **at > began).map(|at| *at - began));
+        took.power.push(*stops.power.get(before).expect("the power is commanded off") - began);
     }
     ends.store(true, Ordering::Relaxed);
     coming.join().expect("no panic");
@@ -268,7 +299,8 @@ fn stops_under(load: Load, name: &str, count: usize) -> Vec<Duration> {
         println!("{computed} recordings were computed meanwhile, {refused} sent away from a full queue");
         assert!(computed > 0 && refused > 0, "{computed} and {refused}");
     }
-    took.sort_unstable();
+    took.train.sort_unstable();
+    took.power.sort_unstable();
     took
 }
 
@@ -286,7 +318,9 @@ fn retried(ask: impl Fn() -> String) -> String {
 #[test]
 fn an_emergency_stop_is_on_the_line_though_a_thousand_connections_say_nothing() {
     let load = Load { idle: 1_200, slow: 50, orders: 4, uploads: 0 };
-    assert_eq!(stops_under(load, "emergency-stop", 2).len(), 2);
+    let took = stops_under(load, "emergency-stop", 2);
+    assert_eq!(took.power.len(), 2);
+    assert!(took.train.first().is_some_and(|first| *first <= took.power[0]), "the train is stopped first");
 }
 
 #[test]
@@ -296,18 +330,20 @@ fn emergency_stop_under_full_load() {
     let full = Load { idle: 5_000, slow: 500, orders: 100, uploads: 12 };
     for load in [nothing, Load { uploads: 12, ..nothing }, Load { uploads: 0, ..full }, full] {
         let took = stops_under(load, "emergency-stop-full", 40);
-        let of = |part: usize| took[(took.len() - 1) * part / 100].as_secs_f64() * 1e3;
         println!(
-            "{} idle, {} slow, {} threads of orders, {} of uploads: first byte on the line after {:.1} ms (median), {:.1} ms (95 %), \
-             {:.1} ms (longest of {})",
-            load.idle,
-            load.slow,
-            load.orders,
-            load.uploads,
-            of(50),
-            of(95),
-            of(100),
-            took.len()
+            "{} idle, {} slow, {} threads of orders, {} of uploads:",
+            load.idle, load.slow, load.orders, load.uploads
         );
+        for (what, took) in [("train", took.train), ("power", took.power)] {
+            assert!(!took.is_empty(), "{what}: no command");
+            let of = |part: usize| took[(took.len() - 1) * part / 100].as_secs_f64() * 1e3;
+            println!(
+                "  {what} off on the line after {:.1} ms (median), {:.1} ms (95 %), {:.1} ms (longest of {})",
+                of(50),
+                of(95),
+                of(100),
+                took.len()
+            );
+        }
     }
 }
