@@ -101,7 +101,10 @@ const LINES = [
   [/^refused `(.*)`: (.*)$/, (_, line, why) => `abgelehnt: \`${line}\`: ${logInGerman(why)}`],
   // Reasons of refused commands.
   [/^something moved that Footplate does not drive: check the track, then enter `power on`, or `place` the train that it is$/, "etwas hat sich bewegt, das Footplate nicht fährt: die Gleise prüfen, dann `power on` eingeben, oder mit `place` sagen, welcher Zug es war"],
-  [/^train (\d+) is stopped for safety until the incident is resolved$/, "Zug $1 steht zur Sicherheit, bis der Vorfall geklärt ist"],
+  [
+    /^train (\d+) is stopped for safety: an earlier message says why and what to do$/,
+    "Zug $1 steht zur Sicherheit: Eine frühere Meldung sagt, warum, und was zu tun ist",
+  ],
   [/^train (\d+) may be on turnout (\d+), which is set for another leg .*$/, "Zug $1 steht vielleicht auf Weiche $2, die nicht so liegt, wie er kam, und auf der er zurück entgleisen würde: erst vorwärts von ihr herunterfahren"],
   [/^the position of train (\d+) would be lost if it reversed here: set `(.+)` first$/, "die Position von Zug $1 ginge verloren, wenn er hier die Richtung wechselte: erst `$2` stellen"],
   [/^sensors report at random$/, "Melder melden wahllos"], [/^sensors report at random: wait until none has for 3 s, then enter it again$/, "Melder melden wahllos: warten, bis 3 s lang keiner meldet, dann noch einmal eingeben"],

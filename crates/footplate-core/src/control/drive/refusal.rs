@@ -246,7 +246,7 @@ impl fmt::Display for Refusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::InDanger { train } => {
-                write!(f, "train {train} is stopped for safety until the incident is resolved")
+                write!(f, "train {train} is stopped for safety: an earlier message says why and what to do")
             }
             Self::TrackNotClear => f.write_str(
                 "something moved that Footplate does not drive: check the track, then enter `power on`, or `place` the train that it is",
