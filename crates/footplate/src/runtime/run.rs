@@ -348,9 +348,10 @@ impl<'r, L: Link> Runtime<'r, L> {
 
     /// Lets the guardian know that no train is left to stop.
     fn release_guardian(&mut self) -> Result<(), Lost> {
-        let is_complete = self.session.closing().is_complete();
+        let closing = self.session.closing();
+        let is_complete = closing.is_complete();
         if !is_complete && self.link.is_without_guardian() {
-            let lost = format!("{}; all of it is commanded again", self.session.closing());
+            let lost = format!("{closing}; all of it is commanded again");
             say!("{lost}");
             return Err(Lost(lost));
         }

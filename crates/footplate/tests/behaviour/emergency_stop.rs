@@ -18,11 +18,9 @@ use crate::guardian::{child_of, signal};
 use crate::station::Standing;
 use crate::uploads::upload;
 
-/// How a command to the train begins, and one that stops it, the first that an emergency stop sends.
+/// How a command to the train begins (the question `<t 24>` does not), and one that stops it, the first that an emergency stop sends.
 const DRIVE: &[u8] = b"<t 24 ";
 const STOP: &[u8] = b"<t 24 0 ";
-/// `<t 24>` asks the board how the train runs.
-const QUESTION: &[u8] = b"<t 24>";
 /// The command that takes the power from the track, the last that it sends.
 const POWER_OFF: &[u8] = b"<0>";
 /// The end of a command.
@@ -93,7 +91,7 @@ impl Tap {
                                 seen.is_running = false;
                                 seen.trains.push(now);
                             }
-                            said if said.starts_with(DRIVE) && said != QUESTION => seen.is_running = true,
+                            said if said.starts_with(DRIVE) => seen.is_running = true,
                             POWER_OFF => seen.power.push(now),
                             _ => {}
                         }
@@ -346,11 +344,11 @@ fn emergency_stop_under_full_load() {
             "{} idle, {} slow, {} threads of orders, {} of uploads:",
             load.idle, load.slow, load.orders, load.uploads
         );
-        for (what, took) in [("train", took.train), ("power", took.power)] {
+        for (what, took) in [("stop of the train", took.train), ("power off", took.power)] {
             assert!(!took.is_empty(), "{what}: no command");
             let of = |part: usize| took[(took.len() - 1) * part / 100].as_secs_f64() * 1e3;
             println!(
-                "  {what} off on the line after {:.1} ms (median), {:.1} ms (95 %), {:.1} ms (longest of {})",
+                "  {what} on the line after {:.1} ms (median), {:.1} ms (95 %), {:.1} ms (longest of {})",
                 of(50),
                 of(95),
                 of(100),
