@@ -211,7 +211,10 @@ impl Interface {
         // If the reply is lost, the solenoid is released after the silence and the word that follows it.
         let recovery = SILENCE + self.pacing.word_time();
         let request = self.polls.next(now, &self.readings, &self.solenoid, &self.reply_time, recovery)?;
-        Some((request, Purpose::Poll(request)))
+        Some(match self.solenoid.repeat_is_due() {
+            true => (Message::SolenoidOff, Purpose::Release),
+            false => (request, Purpose::Poll(request)),
+        })
     }
 
     fn next_of_closing(&self, now: Timestamp) -> Option<(Message, Purpose)> {

@@ -49,6 +49,22 @@ fn a_solenoid_is_released_through_lost_replies_and_at_the_end() {
     }
 }
 
+/// Nothing answers a release, so that one that is lost is not noticed: every reply may come whole.
+#[test]
+fn a_solenoid_is_released_although_one_byte_or_two_to_the_station_are_lost() {
+    for lost in 0..40 {
+        for apart in 0..4 {
+            let mut bench = Bench::with_cts();
+            bench.run_until(ms(300));
+            bench.say(turnout(11));
+            bench.lose_to_station(&[lost, lost + apart]);
+            bench.run_for(2_000);
+            let held = coil_times(&bench);
+            assert!(held.iter().all(|held| *held <= TimeSpan::from_ms(500)), "{lost}, {apart}: {held:?}");
+        }
+    }
+}
+
 #[test]
 fn a_lost_byte_of_a_command_is_noticed_and_the_command_said_again() {
     for place in 0..2 {

@@ -89,6 +89,7 @@ impl Interface {
         self.output.extend(answers.map(Transmit::Notice));
         self.unanswered.clear();
         self.recovery.answered();
+        self.solenoid.answered();
         self.pacing.answered();
         self.exchange = Exchange::Free;
         true
