@@ -1,8 +1,10 @@
-//! Reversing by hand: refused where the train would derail or its position be lost.
+//! Reversing: refused to a person where the train would derail or its position be lost, and avoided by journeys.
+#![expect(clippy::expect_used, clippy::indexing_slicing, reason = "a test may stop at the first surprise")]
 
-use footplate_core::control::{Dispatcher, Driver, Order, Refusal};
+use footplate_core::control::{Dispatcher, Driver, Order, OrderId, Refusal};
 use footplate_core::track::Leg;
-use footplate_core::{SpeedStep, TurnoutId};
+use footplate_core::tracking::PathPoint;
+use footplate_core::{Command, Length, SpeedStep, TurnoutId};
 
 use crate::dispatching::{STARTS, TRAINS, Traffic, model};
 use crate::toy_railway::{step, straight};
@@ -38,26 +40,65 @@ fn a_train_before_points_that_are_set_against_it_is_not_reversed_by_hand() {
     assert!(traffic.dispatcher.driver().locate(train, traffic.world.now).is_some());
 }
 
-#[test]
-fn a_train_on_points_that_it_pushed_over_is_not_reversed_by_hand() {
-    // Given a train that ran by hand over turnout 2 from its curved leg, while it was set straight, and stopped 30 mm
-    // beyond it: its rear, at least 80 mm behind, is still on it.
+/// A train that ran by hand over turnout 2 from its curved leg, while it was set straight, and stopped 30 mm
+/// beyond it: its rear, at least 80 mm behind, is still on it. No sensor has reported it.
+fn on_points_that_it_pushed_over() -> Traffic {
     let mut traffic = Traffic::with(Dispatcher::watched, [("EN1", 150.0), ("C1", 100.0)]);
     let train = TRAINS[1];
-    let order = |traffic: &mut Traffic, order| traffic.dispatcher.order(traffic.world.now, order);
-    order(&mut traffic, Order::Speed { train, step: step(5) }).expect("a step");
+    by_hand(&mut traffic, Order::Speed { train, step: step(5) }).expect("a step");
     while traffic.world.trains[1].at.offset.as_mm() < 380.0 {
         traffic.run(0.02);
     }
-    order(&mut traffic, Order::Speed { train, step: SpeedStep::STAND }).expect("a step");
+    by_hand(&mut traffic, Order::Speed { train, step: SpeedStep::STAND }).expect("a step");
     traffic.run(4.0);
-    // then it is not reversed, until it has run off the turnout.
+    traffic
+}
+
+fn by_hand(traffic: &mut Traffic, order: Order) -> Result<OrderId, Refusal> {
+    traffic.dispatcher.order(traffic.world.now, order)
+}
+
+#[test]
+fn a_train_placed_on_points_that_it_pushed_over_is_not_reversed_by_a_journey() {
+    // Given a train on points that it pushed over, of which a person says where its end is, and not over which leg it came,
+    let mut traffic = on_points_that_it_pushed_over();
+    let train = TRAINS[1];
+    let (now, layout) = (traffic.world.now, &traffic.world.layout);
+    let at = traffic.world.trains[1].at;
+    let from = layout.edge(at.edge).expect("an edge").from;
+    traffic.dispatcher.place(
+        now,
+        train,
+        PathPoint { node: from, distance: at.offset },
+        Length::from_mm(10.0),
+    );
+    // when it is sent back to where it came from,
+    traffic.go(train, "C2");
+    let is_reversed = |traffic: &Traffic| {
+        let reverses = |(_, command): &(_, Command)| *command == Command::Reverse { train };
+        traffic.world.commands.iter().any(reverses)
+    };
+    let passes = traffic.world.passes.len();
+    let goes_on = |traffic: &Traffic| traffic.wrongs.is_empty() && traffic.world.passes.len() == passes;
+    while goes_on(&traffic) && !is_reversed(&traffic) {
+        traffic.run(0.5);
+    }
+    // then it runs on ahead to the next sensor first, on track that is reserved for it over both legs until then.
+    assert!(!is_reversed(&traffic), "{:#?}", traffic.notices);
+    assert_eq!(traffic.wrongs, Vec::<String>::new());
+}
+
+#[test]
+fn a_train_on_points_that_it_pushed_over_is_not_reversed_by_hand() {
+    let mut traffic = on_points_that_it_pushed_over();
+    let train = TRAINS[1];
+    // Then it is not reversed, until it has run off the turnout.
     let reverse = Order::Reverse { train, then: SpeedStep::STAND };
-    let refused = order(&mut traffic, reverse);
+    let refused = by_hand(&mut traffic, reverse);
     assert_eq!(refused, Err(Refusal::OnTrailedPoints { train, turnout: TurnoutId(2) }));
-    order(&mut traffic, Order::Speed { train, step: step(5) }).expect("a step");
+    by_hand(&mut traffic, Order::Speed { train, step: step(5) }).expect("a step");
     traffic.run(3.5);
-    order(&mut traffic, Order::Speed { train, step: SpeedStep::STAND }).expect("a step");
+    by_hand(&mut traffic, Order::Speed { train, step: SpeedStep::STAND }).expect("a step");
     traffic.run(4.0);
-    order(&mut traffic, reverse).expect("off the turnout");
+    by_hand(&mut traffic, reverse).expect("off the turnout");
 }

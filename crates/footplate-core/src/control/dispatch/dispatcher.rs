@@ -15,9 +15,7 @@ use crate::tracking::PathPoint;
 use crate::units::Length;
 
 use super::dispatched_train::{Assignment, DispatchedTrain, Journey, State};
-use super::movement_authority::{
-    ClearanceEnvelope, PARKED, TrainLengths, parking_places, standstill_reservation,
-};
+use super::movement_authority::{ClearanceEnvelope, PARKED, TrainLengths, parking_places};
 use super::path::OccupiedPath;
 use super::reservation::{Blocks, Reservation};
 use super::route_setting::TurnoutCommand;
@@ -324,15 +322,8 @@ impl Dispatcher {
         self.release_anchors(now, id);
         let Some(train) = self.trains.get(&id) else { return };
         let Some(place) = self.watchdog.driver().position(id, now) else { return };
-        let envelope = self.envelope(now, train);
         let layout = self.watchdog.driver().layout();
-        let mut reservation = self.reserved(standstill_reservation(
-            layout,
-            self.watchdog.driver().turnouts(),
-            place,
-            &train.occupied,
-            envelope,
-        ));
+        let mut reservation = self.track_under(now, train);
         self.reserve_anchors(now, id, place, &mut reservation);
         // A larger uncertainty takes no track of another train: this train is within its earlier reservation.
         let is_free = self.is_free_for(id, &reservation);

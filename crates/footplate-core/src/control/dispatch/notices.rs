@@ -270,13 +270,22 @@ impl Dispatcher {
         false
     }
 
-    /// The track under a train, wherever it may be by the turnouts whose position is known: over both legs of the others.
+    /// The track under a train, wherever it may be by the turnouts whose position is known: over both legs of the others, and of those
+    /// behind a train that an operator placed where it may stand on points that it pushed over.
     pub(super) fn track_under(&self, now: Timestamp, train: &DispatchedTrain) -> Reservation {
         let driver = self.watchdog.driver();
         let (layout, envelope) = (driver.layout(), self.envelope(now, train));
         if let Some(place) = driver.position(train.id, now) {
             let turnouts = driver.turnouts();
-            let taken = standstill_reservation(layout, turnouts, place, &train.occupied, envelope);
+            let mut taken = standstill_reservation(layout, turnouts, place, &train.occupied, envelope);
+            if self.watchdog.was_placed_on_points(train.id)
+                && let Some(back) = layout.reversed(place)
+            {
+                for (id, left) in layout.edges_within([(back.edge, back.offset + envelope.behind)]) {
+                    let from = if id == back.edge { back.offset } else { Length::ZERO };
+                    taken.take(layout, id, from, left);
+                }
+            }
             return self.reserved(taken);
         }
         let mut taken = Reservation::empty();

@@ -122,7 +122,7 @@ impl Watchdog {
     /// lie.
     pub(super) fn sensor_behind(&self, now: Timestamp, train: TrainId) -> Option<NodeId> {
         let layout = self.driver.layout();
-        let behind = self.behind.get(&train).filter(|_| !self.undirected.contains(&train))?.sensor;
+        let behind = self.behind.get(&train).filter(|_| !self.undirected.contains(&train))?.sensor?;
         let run = self.unheard_run(now, train);
         let closed = self.closed_to(now, train);
         // Without a dispatcher, closed track is under other trains: this one is not beyond it.
@@ -143,28 +143,38 @@ impl Watchdog {
 
     /// Whether a train may stand on points that it pushed over: back over them it would derail.
     pub(super) fn has_pushed_over_points(&self, now: Timestamp, train: TrainId) -> bool {
-        let Some(behind) = self.behind.get(&train) else { return false };
-        let run = self.unheard_run(now, train);
-        let layout = self.driver.layout();
-        let reach = edges_within(layout, behind.sensor, run + BODY, &Reservation::empty());
-        behind.trails_otherwise || reach.keys().any(|edge| self.lies_otherwise(*edge))
+        self.pushed_over(now, train).is_some()
     }
 
-    /// What is behind a train that an operator places: the points that it may have pushed over, if it may stand on them at its
-    /// new place. A person who enters where its end is does not say over which leg it came.
+    /// The edges that a train may have run over since its last detection, or since it was placed or reversed, if points that it pushed
+    /// over may be among them.
+    pub(super) fn pushed_over(&self, now: Timestamp, train: TrainId) -> Option<BTreeMap<EdgeId, Length>> {
+        let reach = self.unheard_run(now, train) + BODY;
+        let layout = self.driver.layout();
+        let behind = self.behind.get(&train);
+        let over = match (behind.and_then(|behind| behind.sensor), self.seen.get(&train)) {
+            (Some(sensor), _) => {
+                layout.edges_within(layout.outgoing(sensor).edges().map(|edge| (edge, reach)))
+            }
+            (None, Some(seen)) => layout.edges_within([(seen.edge, reach + seen.offset)]),
+            (None, None) => BTreeMap::new(),
+        };
+        let trails_otherwise = behind.is_some_and(|behind| behind.trails_otherwise);
+        (trails_otherwise || over.keys().any(|edge| self.lies_otherwise(*edge))).then_some(over)
+    }
+
+    /// What is behind a train that an operator places, if it may have run `over` points that it pushed over and may stand on them
+    /// at its new place. A person who enters where its end is does not say over which leg it came.
     pub(super) fn behind_placed(
         &self,
-        now: Timestamp,
-        train: TrainId,
         place: Position,
         uncertainty: Length,
+        over: &BTreeMap<EdgeId, Length>,
     ) -> Option<Behind> {
-        let behind = self.behind.get(&train).filter(|_| self.has_pushed_over_points(now, train))?;
-        let reach = self.unheard_run(now, train) + BODY;
-        let reach = edges_within(self.driver.layout(), behind.sensor, reach, &Reservation::empty());
         let within = BODY + uncertainty * CERTAIN;
-        (reach.contains_key(&place.edge) && has_points_behind(self.driver.layout(), place, within))
-            .then_some(Behind { trails_otherwise: true, was_placed: true, ..*behind })
+        let may_stand_on_them =
+            over.contains_key(&place.edge) && has_points_behind(self.driver.layout(), place, within);
+        may_stand_on_them.then_some(Behind { sensor: None, trails_otherwise: true, was_placed: true })
     }
 
     /// Whether an operator placed a train where it may stand on points that it pushed over, and no sensor has reported it since.
@@ -182,7 +192,7 @@ impl Watchdog {
 
     /// A train has passed a sensor.
     pub(super) fn note_behind(&mut self, train: TrainId, sensor: NodeId) {
-        let before = self.behind.get(&train).map(|behind| behind.sensor);
+        let before = self.behind.get(&train).and_then(|behind| behind.sensor);
         let trails_otherwise = before.is_some_and(|before| {
             let mut edges: Vec<EdgeId> = Vec::new();
             for hop in self.driver.context().hops_ahead(before).take(MAX_MISSED + 1) {
@@ -199,7 +209,7 @@ impl Watchdog {
             });
             under.any(|edge| self.lies_otherwise(edge))
         });
-        self.behind.insert(train, Behind { sensor, trails_otherwise, was_placed: false });
+        self.behind.insert(train, Behind { sensor: Some(sensor), trails_otherwise, was_placed: false });
     }
 
     /// The longest distance that a train can have run since its last detection.

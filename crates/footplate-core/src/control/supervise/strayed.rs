@@ -100,7 +100,7 @@ impl Watchdog {
             self.undirected.remove(&train);
         }
         self.seen.insert(train, Position { edge, offset: Length::ZERO });
-        self.behind.insert(train, Behind { sensor: node, trails_otherwise: false, was_placed: false });
+        self.behind.insert(train, Behind { sensor: Some(node), trails_otherwise: false, was_placed: false });
         self.note_detection(train, time);
     }
 

@@ -33,8 +33,8 @@ impl Unheard {
 /// What is behind a train.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Behind {
-    /// The sensor that reported it last.
-    pub(super) sensor: NodeId,
+    /// The sensor that reported it last; `None` if it was placed since.
+    pub(super) sensor: Option<NodeId>,
     /// Whether the rear of a train that has just reached the sensor is on points that it pushed over.
     pub(super) trails_otherwise: bool,
     /// Whether an operator has placed the train since, where it may still be on these points.

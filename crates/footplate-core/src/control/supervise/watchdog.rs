@@ -159,13 +159,12 @@ impl Watchdog {
     /// cancelled.
     pub fn place(&mut self, now: Timestamp, train: TrainId, at: PathPoint, uncertainty: Length) {
         // A recovery that was given up is forgotten, and what the train pushed over is not.
-        let behind = self.behind.get(&train).copied();
+        let over = self.pushed_over(now, train);
         self.end_search(now, train);
-        self.behind.extend(behind.map(|behind| (train, behind)));
         self.driver.place(now, train, at, uncertainty);
         self.monitors.entry(train).or_default().place();
         let place = self.driver.position(train, now);
-        let behind = place.and_then(|place| self.behind_placed(now, train, place, uncertainty));
+        let behind = place.zip(over).and_then(|(place, over)| self.behind_placed(place, uncertainty, &over));
         self.note_place(now, train);
         self.note_detection(train, now);
         self.behind.remove(&train);
