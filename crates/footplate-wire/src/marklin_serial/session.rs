@@ -262,7 +262,8 @@ impl Interface {
         match sending.purpose {
             Purpose::Recovery => {}
             Purpose::Release => {
-                if let Some((turnout, held)) = self.solenoid.release(at) {
+                let is_noisy = self.silence.is_noisy(at);
+                if let Some((turnout, held)) = self.solenoid.release(at, is_noisy) {
                     self.notify(LinkNotice::SolenoidLate { turnout, held });
                 }
                 self.farewell.released = self.farewell.begun;

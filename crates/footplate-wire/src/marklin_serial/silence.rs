@@ -17,6 +17,9 @@ const GARBLED: usize = 3;
 const GARBLED_WITHIN: TimeSpan = TimeSpan::from_ms(5_000);
 /// A line is clean again when none has come for this time.
 const CLEAN_FOR: TimeSpan = TimeSpan::from_ms(3_000);
+/// For so long after a reply was lost or garbled, single bytes to the station may be altered, too, unnoticed: noise that alters one byte
+/// in 300 leaves 170 replies, which come in that time, whole once in 500 times.
+const NOISY_FOR: TimeSpan = TimeSpan::from_ms(10_000);
 
 /// The watch over the station's answers.
 #[derive(Debug, Clone, Default)]
@@ -27,6 +30,8 @@ pub(super) struct Silence {
     bytes: usize,
     /// When replies last came garbled, the newest last.
     garbled: [Option<Timestamp>; GARBLED],
+    /// When a reply was last lost or garbled.
+    disturbed: Option<Timestamp>,
     /// What was said of it last.
     said: Option<Said>,
 }
@@ -47,8 +52,14 @@ impl Silence {
         self.bytes = self.bytes.saturating_add(bytes);
     }
 
+    /// Whether a single byte to the station may be altered without any other sign.
+    pub(super) fn is_noisy(&self, now: Timestamp) -> bool {
+        self.disturbed.is_some_and(|at| now - at < NOISY_FOR)
+    }
+
     /// A reply came garbled; says so when it is one of many.
     pub(super) fn garbled(&mut self, now: Timestamp) -> Option<LinkNotice> {
+        self.disturbed = Some(now);
         self.garbled.rotate_left(1);
         if let Some(newest) = self.garbled.last_mut() {
             *newest = Some(now);
@@ -80,6 +91,7 @@ impl Silence {
 
     /// A reply was lost; says so when it is the last straw.
     pub(super) fn lost(&mut self, now: Timestamp) -> Option<LinkNotice> {
+        self.disturbed = Some(now);
         if self.lost == 0 {
             // The station may have fallen silent in the middle of a reply.
             self.bytes = 0;

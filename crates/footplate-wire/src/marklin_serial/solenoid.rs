@@ -12,8 +12,9 @@ const HOLD: TimeSpan = TimeSpan::from_ms(150);
 /// line is in step.
 const HURRY_AFTER: TimeSpan = TimeSpan::from_ms(250);
 
-/// How often a release is repeated, once after each of the next whole replies. Nothing confirms it: where noise alters its one byte,
-/// every reply may still come whole. Three releases are altered once in 8000 times where one byte in twenty is.
+/// How often a release is repeated on a line that was disturbed, once after each of the next whole replies. Nothing confirms it: where
+/// noise alters its one byte, every reply may still come whole. Three releases are altered once in 8000 times where one byte in
+/// twenty is.
 const REPEATS: u8 = 2;
 
 /// The solenoid that is powered, if one is, and how often the last release is still to be repeated.
@@ -31,9 +32,13 @@ impl Solenoid {
         *self = Self { powered: Some((turnout, at)), ..Self::default() };
     }
 
-    /// It was released; returns what was powered for longer than it bears.
-    pub(super) fn release(&mut self, at: Timestamp) -> Option<(TurnoutId, TimeSpan)> {
-        self.repeats = if self.is_powered() { REPEATS } else { self.repeats.saturating_sub(1) };
+    /// It was released, on a line that may be noisy or not; returns what was powered for longer than it bears.
+    pub(super) fn release(&mut self, at: Timestamp, is_noisy: bool) -> Option<(TurnoutId, TimeSpan)> {
+        self.repeats = match self.powered {
+            Some(_) if is_noisy => REPEATS,
+            Some(_) => 0,
+            None => self.repeats.saturating_sub(1),
+        };
         self.repeat_is_due = false;
         let (turnout, since) = self.powered.take()?;
         let held = at - since;

@@ -49,13 +49,16 @@ fn a_solenoid_is_released_through_lost_replies_and_at_the_end() {
     }
 }
 
-/// Nothing answers a release, so that one that is lost is not noticed: every reply may come whole.
+/// Nothing answers a release, so that one that is lost is not noticed: every reply may come whole. On a line that has lost a
+/// byte it is repeated.
 #[test]
 fn a_solenoid_is_released_although_one_byte_or_two_to_the_station_are_lost() {
     for lost in 0..40 {
         for apart in 0..4 {
             let mut bench = Bench::with_cts();
             bench.run_until(ms(300));
+            bench.lose_to_host(&[0]);
+            bench.run_for(500);
             bench.say(turnout(11));
             bench.lose_to_station(&[lost, lost + apart]);
             bench.run_for(2_000);
