@@ -31,8 +31,8 @@ export const ERRORS = [
   // Requests.
   [/^too many orders wait: .*$/, "zu viele Befehle warten: gleich noch einmal versuchen"], [/^the control loop did not answer: .*$/, "die Steuerschleife hat nicht geantwortet: ist die Verbindung in Ordnung?"],
   [/^the request did not arrive within (\S+) s: .*$/, "die Anfrage ist in $1 s nicht angekommen: noch einmal senden"],
-  [/^too many requests are being computed: .*$/, "zu viele Anfragen werden berechnet: gleich noch einmal versuchen"], [/^the recording did not arrive within (\S+) s$/, "die Aufzeichnung ist in $1 s nicht angekommen"],
-  [/^the recording is too large: at most (\S+) MB are allowed$/, "die Aufzeichnung ist zu groß: höchstens $1 MB sind erlaubt"], [/^this session has no store: .*$/, "diese Sitzung hat keinen Speicher: sie mit `--store railway.db` beginnen"],
+  [/^too many requests are being computed: .*$/, "zu viele Anfragen werden berechnet: gleich noch einmal versuchen"], [/^what was sent did not arrive within (\S+) s$/, "das Gesendete ist in $1 s nicht angekommen"],
+  [/^what was sent is too large: at most (\S+) MB are allowed$/, "das Gesendete ist zu groß: höchstens $1 MB sind erlaubt"], [/^this session has no store: .*$/, "diese Sitzung hat keinen Speicher: sie mit `--store railway.db` beginnen"],
   [/^this page has been dropped: .*$/, "diese Seite ist nicht mehr da: die Aufzeichnung noch einmal senden"], [/^four slides are being watched already: .*$/, "vier Rutschfahrten laufen schon: in einer Minute noch einmal versuchen"],
   // The set-up.
   [/^choose a command station first$/, "erst eine Zentrale wählen"], [/^choose or draw a layout first$/, "erst eine Anlage wählen oder zeichnen"], [/^name a train first$/, "erst einen Zug nennen"],

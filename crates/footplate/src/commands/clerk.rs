@@ -10,9 +10,10 @@ use std::process::ExitStatus;
 use clap::Args;
 use footplate_store::Store;
 use serde::{Deserialize, Serialize};
+use serde_json::json;
 
 use super::Outcome;
-use super::dashboard_routes::{AnswerForm, StoreQuery};
+use super::dashboard_routes::{AnswerForm, DrawnLayout, StoreQuery};
 use super::odometry::uploaded_page;
 use super::written_layout::WrittenLayout;
 
@@ -50,6 +51,8 @@ pub(crate) enum Question {
         layout: String,
         query: StoreQuery,
     },
+    /// Whether the layout that follows, `{"toml": ".."}`, is sound.
+    DrawnLayout,
 }
 
 impl Arguments {
@@ -66,6 +69,10 @@ impl Arguments {
                 let layout = WrittenLayout::of("the session's layout", layout)?.layout;
                 let store = if query.writes() { Store::open(&path)? } else { Store::open_to_read(&path)? };
                 query.answer(&layout, store)?
+            }
+            Question::DrawnLayout => {
+                serde_json::from_reader::<_, DrawnLayout>(&mut input)?.written()?;
+                json!({ "taken": true }).to_string()
             }
         };
         output.write_all(answer.as_bytes())?;

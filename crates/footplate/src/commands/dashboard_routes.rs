@@ -21,7 +21,7 @@ use crate::standard_error::say;
 pub(crate) use answer_queue::{AnswerForm, AnswerQueue};
 pub(crate) use archive::StoreQuery;
 pub(super) use archive::{Archive, archive_routes};
-pub(super) use drawn_layout::drawn_layout_routes;
+pub(super) use drawn_layout::{DrawnLayout, drawn_layout_routes};
 use odometry_pages::odometry_routes;
 pub(super) use schedules::schedule_routes;
 #[cfg(test)]
@@ -57,7 +57,7 @@ fn session_routes(archive: Archive, answer_queue: &AnswerQueue, board: &Arc<Boar
         .and(schedule_routes(archive, Arc::clone(board)))
         .and(odometry_routes(answer_queue))
         .and(slide_routes())
-        .and(drawn_layout_routes())
+        .and(drawn_layout_routes(answer_queue))
 }
 
 /// The same for the test of the description.

@@ -411,6 +411,8 @@ pub(crate) fn answered(answer: Result<Option<String>, NotDone>) -> Response {
 mod tests {
     use std::collections::BTreeSet;
 
+    use hyper_util::service::TowerToHyperService;
+
     use super::*;
     use crate::commands::{session_paths, set_up_paths};
 
@@ -428,9 +430,34 @@ mod tests {
     }
 
     #[test]
+    fn a_wrong_token_is_answered_late_and_an_encoded_one_is_right() {
+        let text = "a-token+of/letters=";
+        let guard =
+            || Guard::new(ServedAt::USUAL.0, Some(Token::chosen(text).expect("a token that is long enough")));
+        let shared = || Shared { board: Board::new(0), layout: "".into(), line: SharedTallies::default() };
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_time().build().expect("a runtime");
+        let ask = |path: &str| {
+            let service = TowerToHyperService::new(router(guard(), own_routes(shared())));
+            let request = Request::get(path).header(header::HOST, ServedAt::USUAL.0.to_string());
+            let began = tokio::time::Instant::now();
+            let answer = runtime
+                .block_on(hyper::service::Service::call(
+                    &service,
+                    request.body(axum::body::Body::empty()).expect("a request"),
+                ))
+                .expect("an answer");
+            assert_eq!(answer.headers()[header::X_CONTENT_TYPE_OPTIONS], "nosniff", "{path}");
+            (answer.status(), began.elapsed() >= WRONG_TOKEN_DELAY)
+        };
+        assert_eq!(ask("/api/picture?token=a-token%2Bof%2Fletters%3D"), (StatusCode::OK, false));
+        assert_eq!(ask("/api/picture?token=a-token%2Bof%2Fletters"), (StatusCode::UNAUTHORIZED, true));
+        assert_eq!(ask("/api/picture"), (StatusCode::UNAUTHORIZED, true));
+    }
+
+    #[test]
     fn every_path_that_takes_a_body_is_fuzzed_from_an_example() {
-        // Answered by another process: what reads recordings has targets of its own, and the doctor takes nothing.
-        const OF_OTHERS: [&str; 2] = ["/api/odometry/{name}", "/api/setup/doctor"];
+        // Answered by another process: what reads recordings and layouts has targets of its own, and the doctor takes nothing.
+        const OF_OTHERS: [&str; 3] = ["/api/odometry/{name}", "/api/setup/doctor", "/api/layout/check"];
         let described: serde_json::Value = serde_json::from_str(OPENAPI).expect("JSON");
         let takes = described["paths"].as_object().expect("paths").iter();
         let takes: BTreeSet<String> = takes

@@ -98,3 +98,41 @@ fn a_calibration_that_is_killed_leaves_the_beginning_of_the_one_that_is_not() {
         assert!(next.status < 2 && next.errors.contains("going on from 1 run "), "{}", next.errors);
     }
 }
+
+/// How far behind the session the disk is, of a train that runs and is given an order every 50 ms.
+#[cfg(unix)]
+#[test]
+#[ignore = "a measurement, for docs/trust.md"]
+fn how_far_the_store_lags_behind_the_session() {
+    use std::io::{Read as _, Write as _};
+    use std::net::TcpStream;
+    use std::time::Duration;
+
+    const ORDERS: u32 = 400;
+    let (_board, _line, driven, _) = crate::guardian::running("lag-on-disk");
+    let host = driven.host();
+    let mut lags_ms: Vec<f64> = Vec::new();
+    for nth in 0..ORDERS {
+        driven.order(&format!("speed 24 {}", 5 + nth % 9));
+        for _ in 0..5 {
+            let mut stream = TcpStream::connect(&host).expect("a connection");
+            write!(stream, "GET /api/picture HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n")
+                .expect("sent");
+            let mut answer = String::new();
+            stream.read_to_string(&mut answer).expect("an answer");
+            let (_, body) = answer.split_once("\r\n\r\n").expect("a body");
+            let picture: serde_json::Value = serde_json::from_str(body).expect("JSON");
+            let time = |key: &str| picture[key].as_f64();
+            lags_ms
+                .extend(time("t_s").zip(time("written_until_s")).map(|(now, written)| 1e3 * (now - written)));
+            thread::sleep(Duration::from_millis(10));
+        }
+    }
+    lags_ms.sort_by(f64::total_cmp);
+    let at = |share: f64| lags_ms[((lags_ms.len() - 1) as f64 * share) as usize];
+    let [median, most, nearly_all, longest] = [0.5, 0.95, 0.99, 1.0].map(at);
+    println!(
+        "{} pictures: behind by {median:.0} ms (median), {most:.0} (95 %), {nearly_all:.0} (99 %), {longest:.0} (longest)",
+        lags_ms.len()
+    );
+}

@@ -68,15 +68,19 @@ fn send(host: &str, name: &str, recording: &[u8]) -> String {
 
 /// Uploads a recording; returns the answer.
 pub(crate) fn upload(host: &str, name: &str, recording: &[u8]) -> std::io::Result<String> {
+    post(host, &format!("/api/odometry/{name}"), recording)
+}
+
+fn post(host: &str, path: &str, body: &[u8]) -> std::io::Result<String> {
     let mut stream = TcpStream::connect(host)?;
     stream.set_read_timeout(Some(PATIENCE))?;
-    let length = recording.len();
+    let length = body.len();
     write!(
         stream,
-        "POST /api/odometry/{name} HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\nContent-Type: application/octet-stream\r\nContent-Length: {length}\r\n\r\n"
+        "POST {path} HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\nContent-Type: application/octet-stream\r\nContent-Length: {length}\r\n\r\n"
     )?;
     // A server that refuses need not read to the end.
-    let _ = stream.write_all(recording);
+    let _ = stream.write_all(body);
     let mut answer = Vec::new();
     let _ = stream.read_to_end(&mut answer);
     Ok(String::from_utf8_lossy(&answer).into_owned())
@@ -107,6 +111,14 @@ fn a_recording_that_grows_without_end_is_refused_and_the_program_lives_on() {
     }
     let after = memory_kb(driven.child(), "VmHWM:");
     println!("the program: {before} kB at most before, {after} kB after");
+    assert!(after < before + PASSED_ON_KB, "{before} kB, then {after} kB");
+    // A layout of 45 000 tables, which takes 190 MB to read.
+    let tables: String = (0..45_000).map(|nth| format!("a{nth}.b.c.d=1\n")).collect();
+    let layout = serde_json::json!({ "toml": tables }).to_string();
+    let answer = post(&host, "/api/layout/check", layout.as_bytes()).expect("sent");
+    assert!(answer.contains("422") && answer.contains("the drawn layout"), "{answer}");
+    let after = memory_kb(driven.child(), "VmHWM:");
+    println!("the program after a layout: {after} kB");
     assert!(after < before + PASSED_ON_KB, "{before} kB, then {after} kB");
     // Many at once wait, or are sent away.
     let runs = Arc::new(short_runs());

@@ -56,9 +56,9 @@ impl AnswerQueue {
         Self { permits: Arc::new(Semaphore::new(MAX_REQUESTS)), turn: Arc::new(Semaphore::new(1)) }
     }
 
-    /// Computes an answer as JSON, or the reason why not.
-    pub(super) async fn answer(&self, question: Question) -> Response {
-        match self.ask(question, Body::empty(), 0).await {
+    /// Computes the answer to a request with a body of at most `most` bytes as JSON, or the reason why not.
+    pub(super) async fn answer(&self, question: Question, body: Body, most: usize) -> Response {
+        match self.ask(question, body, most).await {
             Ok(text) => {
                 ([(header::CONTENT_TYPE, "application/json"), (header::CACHE_CONTROL, "no-store")], text)
                     .into_response()
@@ -92,7 +92,7 @@ impl AnswerQueue {
             answer
         });
         let sent = timeout(UPLOAD_TIMEOUT, forward_body(body, most, &parts)).await.unwrap_or_else(|_| {
-            let why = format!("the recording did not arrive within {} s", UPLOAD_TIMEOUT.as_secs());
+            let why = format!("what was sent did not arrive within {} s", UPLOAD_TIMEOUT.as_secs());
             Err(Rejection(StatusCode::REQUEST_TIMEOUT, why))
         });
         if sent.is_err() {
@@ -119,7 +119,7 @@ async fn forward_body(body: Body, most: usize, parts: &mpsc::Sender<BodyPart>) -
         let part = part.map_err(|error| Rejection(StatusCode::BAD_REQUEST, error.to_string()))?;
         count += part.len();
         if count > most {
-            let why = format!("the recording is too large: at most {} MB are allowed", most >> 20);
+            let why = format!("what was sent is too large: at most {} MB are allowed", most >> 20);
             return Err(Rejection(StatusCode::PAYLOAD_TOO_LARGE, why));
         }
         if parts.send(BodyPart::Bytes(part)).await.is_err() {

@@ -84,7 +84,7 @@ impl Archive {
 
     pub(super) async fn answer(&self, query: StoreQuery) -> Response {
         match self.question(query) {
-            Ok(question) => self.answer_queue.answer(question).await,
+            Ok(question) => self.answer_queue.answer(question, Body::empty(), 0).await,
             Err(rejection) => rejection.into_response(),
         }
     }

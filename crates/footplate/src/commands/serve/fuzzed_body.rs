@@ -13,14 +13,13 @@ use hyper_util::service::TowerToHyperService;
 use serde_json::Value;
 
 use crate::commands::dashboard_routes::{
-    AnswerQueue, Archive, SetUpRoute, archive_routes, drawn_layout_routes, fuzzed_set_up_routes,
-    schedule_routes,
+    AnswerQueue, Archive, SetUpRoute, archive_routes, fuzzed_set_up_routes, schedule_routes,
 };
 use crate::commands::drive::FuzzedSession;
 use crate::dashboard::{Routes, answering, driving_routes};
 
 /// Paths that answer by starting the program again; the fuzzer is not the program.
-const STARTS_A_PROCESS: [&str; 1] = ["/api/setup/doctor"];
+const STARTS_A_PROCESS: [&str; 2] = ["/api/setup/doctor", "/api/layout/check"];
 /// The longest answer.
 const LONGEST_ANSWER: usize = 1 << 20;
 
@@ -78,7 +77,6 @@ fn routes(path: &str, session: &FuzzedSession, folder: &Folder) -> anyhow::Resul
     Ok(driving_routes(&session.board, &file)?
         .and(archive_routes(archive.clone()))
         .and(schedule_routes(archive, Arc::clone(&session.board)))
-        .and(drawn_layout_routes())
         .and(SetUpRoute::fixed().routes()))
 }
 
