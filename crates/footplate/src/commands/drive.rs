@@ -62,9 +62,9 @@ use crate::standard_error::say;
 /// Drive trains: speeds, turnouts, exact stops, moves, following.
 ///
 /// Without `--script`, commands are read from standard input, one a line; at a terminal there is a prompt, and a new
-/// command replaces the train's previous one. With `--serve` they are read at a terminal only: others send them over HTTP. `help` lists the commands. The program prints each detection beside its
-/// prediction, and each stop beside its predicted interval. However the program ends, it first commands all trains to
-/// stop and switches the track power off.
+/// command replaces the train's previous one. With `--serve` they are read at a terminal only: others send them over
+/// HTTP. `help` lists the commands. The program prints each detection beside its prediction, and each stop beside its
+/// predicted interval. However the program ends, it first commands all trains to stop and switches the track power off.
 #[derive(Args)]
 #[command(mut_arg("link", |link| link.required(true)), after_help = "\
 Examples:

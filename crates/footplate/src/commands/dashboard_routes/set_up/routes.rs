@@ -28,8 +28,7 @@ use footplate_store::{BUILT_IN, built_in, write_whole};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use super::super::answer_queue::AnswerQueue;
-use super::super::answer_queue::Rejection;
+use super::super::answer_queue::{AnswerQueue, Rejection};
 use super::super::drawn_layout::{DrawnLayout, LARGEST_LAYOUT, drawn_layout_routes};
 use super::set_up_file::{SetUp, SetUpTrain, StepResult};
 use super::{Next, check_link};
